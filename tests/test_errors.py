@@ -34,6 +34,8 @@ def test_a_long_list_of_names_is_cut_but_the_nearest_is_always_named():
     assert text.startswith("did you mean 'link_")
     assert text.endswith("and 488 more")
     assert "link_437" in suggestion("link_437x", names)
+    of_the_arm = suggestion("arm/tool0", [*names, "arm/zulu", "arm/flange"])
+    assert of_the_arm.startswith("known: arm/flange, arm/zulu, link_000")
     assert suggestion("zzz", names).startswith("known: link_000")
 
 

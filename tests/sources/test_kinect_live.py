@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import seerob as sr
 from free_ports import free_port
 from reached import reached
 from seerob.app.emulators.kinect import CAMERA, KinectSender, animated
@@ -25,6 +26,7 @@ from seerob.protocols.tracking.kinect import (
     decode_message,
     encode_message,
 )
+from seerob.session.opening import open_sources
 from seerob.workstation.workstation import Pose
 
 PATIENCE = 120.0
@@ -165,6 +167,18 @@ def test_what_is_wrong_with_a_message_is_said(change, message):
     data = msgspec.json.decode(encode_message(Picture(t=1.0, bodies=()))) | change
     with pytest.raises(ProtocolError, match=message):
         decode_message(msgspec.json.encode(data))
+
+
+def test_a_camera_without_a_place_is_named_by_its_table(tmp_path):
+    """The file, and which of its sources: the source knows neither."""
+    (tmp_path / "workstation.toml").write_text(
+        '[[humans]]\nname = "eva"\nstature = 1.7\nmass = 65\nsex = "female"\n'
+        '[[sources]]\nkind = "kinect"\nhuman = "eva"\n'
+    )
+    with pytest.raises(InputError) as caught:
+        open_sources(sr.load(tmp_path).model)
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.key) == ("workstation.toml", "sources[0].at")
 
 
 def test_what_must_be_given_is_asked(tmp_path):

@@ -77,11 +77,15 @@ def ended_by(error: BaseException) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """``did you mean 'ur10'? known: …`` for a wrong name, with at most a dozen of the known ones."""
+    """``did you mean 'ur10'? known: …`` for a wrong name, with at most a dozen of the known ones.
+
+    Of a name with an owner, ``ur10/tool1``, those of the same owner come first.
+    """
     known = tuple(known)
     close = get_close_matches(name, known, n=1, cutoff=0.6)
     head = f"did you mean {close[0]!r}? " if close else ""
     if not known:
         return head + "known: none"
-    shown = ", ".join(sorted(known)[:12])
+    owner = name.rpartition("/")[0]
+    shown = ", ".join(sorted(known, key=lambda each: (each.rpartition("/")[0] != owner, each))[:12])
     return head + f"known: {shown}" + (f" and {len(known) - 12} more" if len(known) > 12 else "")

@@ -174,6 +174,15 @@ def given(name: str, value: float, unit: str) -> Input:
     return Input(name=name, value=value, unit=unit, origin=Origin.GIVEN, source="workstation file")
 
 
+def option(name: str, value: float, usual: float, unit: str) -> Input:
+    """A number that the workstation file may give, and that of seerob when it does not."""
+    if value != usual:
+        return given(name, value, unit)
+    shown = f"{usual:g} {unit}"
+    source = f"workstation file, {shown} when not given"
+    return Input(name=name, value=value, unit=unit, origin=Origin.CHOICE, source=source)
+
+
 def limit(value: float | None, unit: str) -> tuple[Input, ...]:
     """The limit that the workstation file gives, if any."""
     return () if value is None else (given("limit", value, unit),)

@@ -317,7 +317,10 @@ def _placed(problem: Problem, source: Source, at: str, file: str) -> Problem:
     """Where the workstation file has what a mistake is about.
 
     That is its name for a data file that cannot be read at all, and waypoints that stand in it themselves.
+    A source knows its own keys, and not the file that has it.
     """
+    if problem.file == "sources":
+        return Problem(file, f"{at}.{problem.key}", problem.what, problem.remedy)
     if isinstance(source, TakesWaypoints) and not getattr(source, "file", ""):
         point = _POINT.search(problem.key)
         key = point[0] if point else problem.key

@@ -51,6 +51,8 @@ FAR = 1e6
 """Larger than any margin of speed [m/s]."""
 GOVERNING = tuple(limit.name.lower() for limit in collision.Governing)
 _BY_RANK = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)
+HORIZON = 0.5
+"""How near a part of a robot must be to hit a body part, when nobody says [m]."""
 CAP = 1e-4
 """Contact area that the stiffness of the table is good for [m²] (STIMBA PFL calculator, 1S)."""
 
@@ -74,7 +76,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     human: str | None = None
     """A person: regions within ``horizon`` of a part can be hit by it, and those of everybody else in the
     workstation. Without one, anyone could stand anywhere."""
-    horizon: _Positive = 0.5
+    horizon: _Positive = HORIZON
     """Distance within which a part of the robot could hit a body part [m]."""
     person_speed: Annotated[float, Meta(ge=0, extra={"unit": "m/s"})] | None = None
     """Speed of the body part, added to the robot's [m/s]; without it as observed, 0 without a person."""
@@ -298,7 +300,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         elif roots:
             found.append(Input(name="drive_force", origin=Origin.MISSING, source=NOT_GIVEN))
         if self.human is not None:
-            found.append(provenance.given("horizon", self.horizon, "m"))
+            found.append(provenance.option("horizon", self.horizon, HORIZON, "m"))
         tolerances = {key: getattr(self, key) for key in ("stiffness_tolerance", "area_tolerance")}
         found += [provenance.given(key, share, "") for key, share in tolerances.items() if share]
         if self.person_speed is not None:

@@ -21,6 +21,8 @@ from seerob.twin.state import State
 
 DRAWN = 2000
 """Triangles of the surface as drawn, about; it still contains every voxel."""
+VOXEL = 0.02
+"""Edge of a voxel, when nobody says [m]."""
 
 
 class SweptVolume(Criterion, frozen=True, kw_only=True):
@@ -32,7 +34,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
 
     of: str
     """What sweeps: a robot with everything on it, a tool, a human, a link; wildcards allowed."""
-    voxel: Annotated[float, Meta(gt=0, extra={"unit": "m"})] = 0.02
+    voxel: Annotated[float, Meta(gt=0, extra={"unit": "m"})] = VOXEL
     """Edge of a voxel [m]."""
     limit: Annotated[float, Meta(ge=0, extra={"unit": "m³"})] | None = None
     """Largest admissible volume [m³]."""
@@ -104,7 +106,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
             inputs=(
                 *provenance.motion(model, *_carriers(model, model.select(self.of))),
                 *(Input(name="shape", value=note, origin=Origin.ESTIMATED, source="model") for note in notes),
-                provenance.given("voxel", self.voxel, "m"),
+                provenance.option("voxel", self.voxel, VOXEL, "m"),
                 *provenance.limit(self.limit, "m³"),
             ),
             not_modelled=tuple(not_modelled),

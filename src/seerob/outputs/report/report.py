@@ -12,8 +12,9 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
-import msgspec
+from msgspec import Struct
 
 from seerob.core import plugin
 from seerob.core.errors import SeerobError, UnknownName
@@ -23,6 +24,7 @@ from seerob.outputs.palette import MARK, WORD
 from seerob.outputs.sentences import number
 from seerob.outputs.words import said, speaking, told, word
 from seerob.recording.result_log import ResultLog
+from seerob.workstation.conversion import convert
 from seerob.workstation.source import Source
 from seerob.workstation.workstation import Engine, ReportCover
 
@@ -121,6 +123,7 @@ def grouped_inputs(items: Iterable[tuple[str, Input]]) -> list[list[str | Html]]
     return found
 
 
+_Table = TypeVar("_Table", bound=Struct)
 UNKNOWN = word("unknown: the workstation file is not at hand or cannot be read")
 ORIGINS = {
     "controller": word("measured: the real robot's controller"),
@@ -159,10 +162,7 @@ def setup(files: dict[str, bytes]) -> Setup:
     if table is None:
         return Setup(((said("physics"), said(UNKNOWN)),), (), readable=False)
     entries = table.get("sources", [])
-    try:
-        cover = msgspec.convert(table.get("report", {}), ReportCover)
-    except msgspec.ValidationError:
-        cover = ReportCover()
+    cover = _read(table.get("report", {}), ReportCover) or ReportCover()
     with speaking(cover.language):
         found = [_source(e) for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
         return Setup(_engine(table.get("engine", {})), tuple(found), readable=True, cover=cover)
@@ -176,10 +176,16 @@ def command() -> str:
     return "a Python program that uses seerob"
 
 
+def _read(table: object, wanted: type[_Table]) -> _Table | None:
+    """A table as the workstation reads it, keys with a unit too; None where it has a mistake."""
+    if not isinstance(table, dict):
+        return None
+    return convert(table, wanted, file="", key="", problems=[])
+
+
 def _engine(table: object) -> tuple[tuple[str, str], ...]:
-    try:
-        e = msgspec.convert(table, Engine, strict=False)
-    except msgspec.ValidationError:
+    e = _read(table, Engine)
+    if e is None:
         return ((said("engine as the file has it"), str(table)),)
     return (
         (
@@ -219,10 +225,10 @@ def _source(entry: dict[str, object]) -> tuple[str, ...]:
         # A report must not import a module because a recording names it.
         if kind not in plugin.kinds("sources"):
             raise UnknownName("kind", kind, ())
-        source = msgspec.convert(rest, plugin.load("sources", kind, Source), strict=False)
-        drives = source.target()
-    except (SeerobError, msgspec.ValidationError, ImportError):
-        source, drives = None, str(rest.get("robot") or rest.get("human") or "")
+        source = _read(rest, plugin.load("sources", kind, Source))
+    except (SeerobError, ImportError):
+        source = None
+    drives = str(rest.get("robot") or rest.get("human") or "") if source is None else source.target()
     name = str(rest.get("name") or f"{kind} {drives}".strip())
     places = [str(rest[key]) for key in _ADDRESSES if key in rest]
     captured = "" if source is None else source.captured

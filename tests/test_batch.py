@@ -248,6 +248,12 @@ def test_who_enters_is_said_of_many_instants_as_of_each(tmp_path, motion, monkey
     assert set(found.answers.verdict.tolist()) == {CODES[verdict] for verdict in verdicts}
     np.testing.assert_array_equal(found.answers.verdict, alone.answers.verdict)
     np.testing.assert_allclose(found.value, alone.value, rtol=1e-12)
+    ends = [one.answers.interval or (one.value, one.value) for one in (found, alone)]
+    np.testing.assert_allclose(*ends, rtol=1e-12)
+    idle = [
+        np.zeros(N, bool) if one.answers.nothing is None else one.answers.nothing for one in (found, alone)
+    ]
+    np.testing.assert_array_equal(*idle)
     said = found.answers.verdict != CODES[Verdict.UNDECIDED]
     np.testing.assert_array_equal(found.reasons[said], alone.reasons[said])
 

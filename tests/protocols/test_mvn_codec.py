@@ -296,6 +296,14 @@ def test_a_recording_that_begins_anew_and_a_counter_that_turns_over():
     assert samples(2**32 - 1, 0, 2**32 - 2) == ([2**32 - 1, 0], 1)
 
 
+def test_a_piece_of_one_recording_is_not_completed_by_the_next():
+    first, second = parts(Kind.QUATERNION, items_each=12, sample=100)
+    later = [data for n in range(100) for data in parts(Kind.QUATERNION, items_each=12, sample=n)]
+    found, losses = fed([first, *later, second])
+    assert [items.header.sample for items in found] == [*range(100)]
+    assert losses.incomplete == 1
+
+
 def test_pieces_that_never_end_take_no_memory():
     assembly = Assembly()
     for sample in range(0, 100_000, 100):

@@ -401,7 +401,13 @@ def _with(
     (answers, reasons), (then, why) = said, again
     picked = {key: np.where(where, getattr(then, key), getattr(answers, key)) for key in ("value", "limit")}
     verdict = np.where(where, then.verdict, answers.verdict).astype(np.uint8)
-    return replace(answers, **picked, verdict=verdict), np.where(where, why, reasons)
+    interval = None
+    if answers.interval is not None or then.interval is not None:
+        ends, others = (one.interval or (one.value, one.value) for one in (answers, then))
+        interval = np.where(where, others[0], ends[0]), np.where(where, others[1], ends[1])
+    nothing = np.where(where, _idle(then), _idle(answers))
+    found = replace(answers, **picked, verdict=verdict, interval=interval, nothing=nothing)
+    return found, np.where(where, why, reasons)
 
 
 def _able(

@@ -461,9 +461,8 @@ class Assembly:
         self._newest[key] = header
         self._waiting.pop((key, header.sample), None)
         if self._waiting:
-            old = [
-                at for at in self._waiting if at[0] == key and (header.sample - at[1]) % _TURN < _TURN // 2
-            ]
+            # Further ahead are pieces of the recording before: its counter comes there again.
+            old = [at for at in self._waiting if at[0] == key and (at[1] - header.sample) % _TURN > LATE]
             for at in old:
                 del self._waiting[at]
                 self.losses.incomplete += 1

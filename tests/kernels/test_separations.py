@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from seerob.criteria.stopping.planned import assumed_speed
-from seerob.criteria.stopping.terms import Course, separation_distance
+from seerob.criteria.stopping.terms import Course, assumed_speed, separation_distance
 from seerob.description.norms.iso_13855 import WALKING, least_distance
 from seerob.kernels.separation import separations
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError, Undecided
-from seerob.criteria.stopping.planned import assumed_speed
+from seerob.criteria.stopping.terms import assumed_speed
 from seerob.description.norms.iso_13855 import (
     Approach,
     Edition,

@@ -25,7 +25,7 @@ from seerob.criteria.safety.effective_mass import inverse_effective_mass, princi
 from seerob.criteria.safety.manipulability import Manipulability, singular_values
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation
-from seerob.criteria.stopping.planned import assumed_speed
+from seerob.criteria.stopping.terms import assumed_speed
 from seerob.description.norms.body_limits import SHIPPED, parse, shipped
 from seerob.description.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance
 from seerob.kernels.separation import approach_speeds

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError, Undecided
-from seerob.criteria.stopping.planned import assumed_speed
 from seerob.criteria.stopping.terms import (
     BOUND,
     CONSTANT,
+    assumed_speed,
     course,
     decelerating,
     largest_factor,

@@ -27,15 +27,7 @@ from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping import many_instants
 from seerob.criteria.stopping.models import MOVING, NOISY, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
-from seerob.criteria.stopping.planned import (
-    OneOf,
-    Stops,
-    assumed_speed,
-    faster,
-    line,
-    permissible,
-    terms,
-)
+from seerob.criteria.stopping.planned import OneOf, Stops, faster, line, permissible, terms
 from seerob.criteria.stopping.reaction import joint_limits
 from seerob.criteria.stopping.required import (
     SIMULATED,
@@ -49,7 +41,7 @@ from seerob.criteria.stopping.required import (
     tolerances,
 )
 from seerob.criteria.stopping.stated_acceleration import JointAccelerations, StatedAcceleration
-from seerob.criteria.stopping.terms import At, Course, way_of_person
+from seerob.criteria.stopping.terms import At, Course, assumed_speed, way_of_person
 from seerob.description.norms.iso_13855 import REACHING, WALKING
 from seerob.distance.least import Closests
 from seerob.kernels.separation import (

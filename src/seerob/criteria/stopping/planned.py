@@ -18,9 +18,10 @@ from seerob.criteria.body_parts import BodyPlaces
 from seerob.criteria.stopping.models import MOVING, StopModel
 from seerob.criteria.stopping.onset import Onset
 from seerob.criteria.stopping.required import TOP
-from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
+from seerob.criteria.stopping.terms import assumed_speed
+from seerob.description.norms.iso_13855 import WALKING
 from seerob.distance.least import Closests, Per
-from seerob.kernels.separation import HumanSpeed, TimedStop, stops_in_time
+from seerob.kernels.separation import TimedStop, stops_in_time
 from seerob.model.model import Gap, Model
 from seerob.recording.series import CODES
 from seerob.twin.state import State
@@ -139,11 +140,6 @@ class _InTime:
     def _where(self, state: State, found: Closests, k: int, seen: float) -> str:
         nearest = self._places.named(state, found.body_a.item(k), found.point_a[k])
         return f"{self._names[k]} ↔ {nearest}{faster(self._one.human, seen, self._one.human_speed)}"
-
-
-def assumed_speed(human_speed: float | None) -> HumanSpeed:
-    """How fast a person is assumed to come: v_h that is given [m/s], or as ISO 13855 has it."""
-    return HumanSpeed(math.nan if human_speed is None else human_speed, REACHING, WALKING, ARM_REACH)
 
 
 def faster(human: str, seen: float, human_speed: float | None) -> str:

@@ -13,6 +13,7 @@ Speeds count as positive whatever their direction, so that what recedes never sh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -21,7 +22,9 @@ from msgspec import Struct
 from seerob.core.domains import at_least, number
 from seerob.core.transforms import Array
 from seerob.criteria.stopping.onset import Onset
+from seerob.description.norms.iso_13855 import ARM_REACH, REACHING, WALKING
 from seerob.kernels import separation as kernel
+from seerob.kernels.separation import HumanSpeed
 from seerob.twin.state import State
 
 BOUND, CONSTANT = 1.0, 0.5
@@ -60,6 +63,11 @@ LEAST = 1e-9
 def _check(**given: float) -> None:
     for name, value in given.items():
         number(name, value, 0)
+
+
+def assumed_speed(human_speed: float | None) -> HumanSpeed:
+    """How fast a person is assumed to come: v_h that is given [m/s], or as ISO 13855 has it."""
+    return HumanSpeed(math.nan if human_speed is None else human_speed, REACHING, WALKING, ARM_REACH)
 
 
 def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, judged, made, state_at, two_r
-from seerob.core.snapshot import Origin
+from seerob.core.snapshot import Origin, Verdict
 from seerob.core.tolerances import Tolerance
 from seerob.criteria.scoring.handled import heavier
 from seerob.description.description import Inertial, rigid
@@ -379,3 +379,26 @@ def test_wherever_mass_is_about_a_known_centre_figures_are_within_their_bounds(t
     )
     sure = made(tmp_path / "given", given, files)
     assert len(MassTolerances(sure.model, sure.model.robot("arm"))) == ends - 1
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_what_has_its_centre_of_mass_beside_its_shape_is_within_nothing_without_inertia(tmp_path, link):
+    """5 cm beside the end of a block: its moments passed for those of nearly a point."""
+    beside = [0.0, 0.0, float(BLOCK[2]) / 2 + 0.05]
+    energy = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 100.0\n'
+    verdicts = []
+    for inertia in ("", "inertia = [0.02, 0.02, 0.005, 0, 0, 0]\n"):
+        files, text = {"arm.urdf": two_r(masses=(0.3, 0.1))}, FLOATING + TWO_R
+        said = f"mass = 2\ncom = {beside}\n{inertia}"
+        if link:
+            files["arm.urdf"] = one("revolute", 0.0).replace("0.1 0.1 0.1", " ".join(map(str, BLOCK)))
+            text += f'[robots.masses.l1]\n{said}source = "a scale"\n'
+        else:
+            text += f'[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ box = {BLOCK.tolist()} }}\n{said}'
+        (tmp_path / f"cell{len(verdicts)}").mkdir()
+        cell = made(tmp_path / f"cell{len(verdicts)}", text + energy, files)
+        n = len(cell.model.robot("arm").joints)
+        found = cell.batch({"arm": np.zeros((1, n))}, {"arm": np.ones((1, n))})["energy"]
+        verdicts.append(found.verdict)
+        assert ("give inertia" in str(found.reasons[0])) == (not inertia)
+    assert verdicts == [Verdict.UNDECIDED, Verdict.WITHIN]

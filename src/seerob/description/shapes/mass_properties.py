@@ -315,18 +315,28 @@ def about_its_centre(
 ) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of what has its centre of mass elsewhere than uniform density has it.
 
-    Its moments are told as those of uniform density, and may be any that a body in that box can have.
+    Its moments are told as those of uniform density, and may be any that a body in that box can have. Where
+    the box does not hold the centre, nothing that depends on the body is within.
 
     Args:
         uniform: At uniform density.
         com: The centre of mass [m].
         box: Lowest and highest corner of one that holds all of it [m].
-        subject: Full name of the body.
+        subject: Full name of the body: its own, or that of its robot and a link's.
     """
     inertial = replace(uniform, com=np.array(com, float))
     off = float(np.linalg.norm(inertial.com - uniform.com))
     if off <= OFF_CENTRE:
         return inertial, ()
+    outside = np.linalg.norm(np.maximum(np.maximum(box[0] - com, com - box[1]), 0.0))
+    if outside > 1e-9:
+        text = (
+            f"its centre of mass is {1e3 * outside:.3g} mm outside the box around its shape, and how mass is "
+            "spread that no shape shows, nobody knows: give inertia"
+        )
+        return inertial, (
+            Finding(level="warning", subject=subject, text=text, holds=(subject.partition("/")[0],)),
+        )
     gyration = max(mass_bounds.largest_gyration(inertial.com, *box), OFF_CENTRE)
     # Those of uniform density may be more than any that has its centre there.
     share = min(1.0, inertial.mass * gyration**2 / float(np.linalg.eigvalsh(inertial.inertia)[-1]))

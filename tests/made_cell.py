@@ -90,6 +90,7 @@ name = "load"
 on = "arm/tool0"
 shape = { box = [0.1, 0.1, 0.1] }
 mass = 3
+uniform_density = true
 tcp = { position = [0, 0, 0.1] }
 """
 Q0, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([1, 0.5, -0.6, 0.8, -0.7, 1.0])

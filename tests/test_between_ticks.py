@@ -26,7 +26,7 @@ from worst_between import one_by_one, worst_found
 msgpack = msgspec.msgpack.Encoder(enc_hook=plain).encode
 
 STICK = (
-    '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.01\n'
+    '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.01\nuniform_density = true\n'
     "shape = { box = [0.1, 0.004, 0.004] }\nat = { position = [0.05, 0, 0] }\n"
 )
 POST = (
@@ -143,7 +143,7 @@ def test_what_a_finding_holds_is_exceeded_between_two_ticks_all_the_same(tmp_pat
     assert Verdict.WITHIN not in found
 
 
-UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong = "motion"\nlimit = 60\n'
+UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\ntoward = "post"\nlimit = 90\n'
 
 
 @pytest.mark.parametrize("accepted", ["", 'between_samples = "accepted: it changes slowly"\n'])

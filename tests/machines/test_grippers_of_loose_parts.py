@@ -15,6 +15,7 @@ ARM = """
 name = "lift"
 shape = { box = [0.1, 0.1, 0.1] }
 mass = 20
+uniform_density = true
 slide = { along = [0, 0, 1] }
 at = { position = [0, 0, 1.23] }
 [[machines]]
@@ -23,6 +24,7 @@ on = "lift"
 at = { position = [0, 0, -0.3] }
 shape = { box = [0.02, 0.01, 0.06] }
 mass = 0.2
+uniform_density = true
 grip = { along = [0, 1, 0], upper = 0.12 }
 [[parts]]
 name = "table"
@@ -34,6 +36,7 @@ BLANK = """
 name = "blank"
 shape = { box = [0.10, 0.05, 0.04] }
 mass = 0.8
+uniform_density = true
 at = { position = [0, 0, 0.821] }
 """
 BOX = """
@@ -142,7 +145,7 @@ def test_what_is_held_may_weigh_more_by_its_tolerance_and_by_what_its_volume_may
     mesh = 'mesh = "blank.stl"\nunits = "m"\ndeviation_mm = 1\n'
     given = BLANK.replace("mass", "mass_tolerance = 0.25\nmass")
     dense = BLANK.replace("shape = { box = [0.10, 0.05, 0.04] }\n", mesh).replace(
-        "mass = 0.8", "density = 4000"
+        "mass = 0.8\nuniform_density = true", "density = 4000"
     )
     for blank, off in ((given, 0.25), (dense, None)):
         cell = Cell(tmp_path, ARM + blank).held().go(60, UP)

@@ -20,6 +20,7 @@ AXIS = """
 name = "axis"
 shape = { box = [0.2, 0.2, 0.1] }
 mass = 5
+uniform_density = true
 turn = { about = [0, 1, 0] }
 [[machines]]
 name = "hand"
@@ -27,6 +28,7 @@ on = "axis"
 at = { position = [1.0, 0, 0] }
 shape = { box = [0.02, 0.02, 0.06] }
 mass = 0.2
+uniform_density = true
 grip = { upper = 0.1 }
 [[parts]]
 name = "post"
@@ -39,6 +41,7 @@ name = "nut"
 on = "hand"
 shape = { box = [0.04, 0.04, 0.04] }
 mass = 2.0
+uniform_density = true
 rest = { position = [1.0, 0, 0.01], rpy = [0.3, 0, 0] }
 """
 STATION = "[engine]\nphysics = false\n" + AXIS + NUT
@@ -194,6 +197,7 @@ SECOND = """
 name = "lift"
 shape = { box = [0.1, 0.1, 0.1] }
 mass = 5
+uniform_density = true
 at = { position = [1.0, 0.5, 0] }
 slide = { along = [0, 0, 1], lower = -1, upper = 1 }
 [[machines]]
@@ -202,6 +206,7 @@ on = "lift"
 at = { position = [0, -0.5, 0] }
 shape = { box = [0.02, 0.02, 0.06] }
 mass = 0.2
+uniform_density = true
 grip = { upper = 0.1, along = [0, 1, 0] }
 """
 
@@ -315,6 +320,7 @@ name = "hand"
 on = "arm/tip"
 shape = { box = [0.02, 0.02, 0.06] }
 mass = 0.2
+uniform_density = true
 grip = { upper = 0.1 }
 """
 WEIGHED = "".join(
@@ -387,12 +393,14 @@ on = "arm/tip"
 at = { position = [0, 0, 0.12] }
 shape = { box = [0.02, 0.02, 0.06] }
 mass = 0.2
+uniform_density = true
 grip = { upper = 0.1 }
 [[workpieces]]
 name = "rod"
 on = "hand"
 shape = { box = [1.6, 0.04, 0.04] }
 mass = 1.0
+uniform_density = true
 rest = { position = [1.2, 0, 0.12] }
 """
 

@@ -55,6 +55,7 @@ def test_one_joint_has_the_moment_of_a_centre_nearer_to_it_or_farther(
     assert [at((side,))[0, 0] for side in (-1, 0, 1)] == pytest.approx([least, nominal, most], abs=1e-12)
 
 
+EVEN = "uniform_density = true\n"
 TOOL = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\n{}\n'
 DENSITY = 0.7 / (4 / 3 * np.pi * 0.02**3)
 
@@ -62,7 +63,7 @@ DENSITY = 0.7 / (4 / 3 * np.pi * 0.02**3)
 @pytest.mark.parametrize("name", ["grip", "arm/grip"])
 def test_links_count_by_half_and_what_is_mounted_in_full_whatever_it_is_called(tmp_path, name):
     """10 % of M/2 = 1 kg, and 10 % of the tool's 3 kg."""
-    tool = TOOL.replace("grip", name).format("mass = 3\nmass_tolerance = 0.1")
+    tool = TOOL.replace("grip", name).format(f"mass = 3\n{EVEN}mass_tolerance = 0.1")
     cell = made(tmp_path, FLOATING + TWO_R + "mass_tolerance = 0.1\n" + tool, {"arm.urdf": two_r()})
     found = MassTolerances(cell.model, cell.model.robot("arm"))
     assert [found.simplified(4.0, shifts) for shifts in ((1, 0), (0, 1))] == pytest.approx([4.1, 4.3])
@@ -117,8 +118,8 @@ def tool_cells(tmp_path_factory):
     cells = []
     for k, (mass, shares) in enumerate(
         [
-            ("mass = 0.7", {}),
-            ("mass = 0.7", {"mass_tolerance": 0.2}),
+            (f"mass = 0.7\n{EVEN}", {}),
+            (f"mass = 0.7\n{EVEN}", {"mass_tolerance": 0.2}),
             (f"density = {DENSITY}", {"density_tolerance": 0.3}),
         ]
     ):
@@ -131,7 +132,7 @@ def tool_cells(tmp_path_factory):
 
 def test_a_bound_that_no_robot_can_have_gives_way_to_one_without_the_body(tmp_path):
     """A heavy grip on light links that may be 0.6 m off: the lesser of the first bounds has no inverse."""
-    text = FLOATING + TWO_R + TOOL.format("mass = 3\ncom_tolerance = 0.6")
+    text = FLOATING + TWO_R + TOOL.format(f"mass = 3\n{EVEN}com_tolerance = 0.6")
     cell = made(tmp_path, text, {"arm.urdf": two_r(masses=(0.1, 0.1))})
     state = state_at(cell, arm=((0.2, 0.3), (1.0, -1.2)))
     plain = state.mass_matrix(cell.model.robot("arm"))
@@ -155,7 +156,7 @@ def test_a_link_that_is_heavier_has_more_of_its_own_inertia_too(tmp_path):
 
 def test_bodies_weigh_what_their_own_tolerances_say_and_no_other(tmp_path):
     """A grip of 3 kg ± 20 % on links ± 10 %, its centre within 2 cm: factors, ways, and the shifted model."""
-    tool = TOOL.format("mass = 3\nmass_tolerance = 0.2\ncom_tolerance = 0.02")
+    tool = TOOL.format(f"mass = 3\n{EVEN}mass_tolerance = 0.2\ncom_tolerance = 0.02")
     other = '[[parts]]\nname = "post"\nshape = { sphere = 0.1 }\nat = { position = [9, 0, 0] }\nmass = 1\n'
     text = FLOATING + TWO_R + "mass_tolerance = 0.1\n" + tool + other
     cell = made(tmp_path, text, {"arm.urdf": two_r()})
@@ -305,7 +306,8 @@ def test_of_a_body_that_several_inputs_leave_open_no_less_is_left_than_nothing(t
     """Its centre may be elsewhere, and so may its surface: together more than it weighs."""
     box = trimesh.creation.box((0.05, 0.05, 0.05)).export(file_type="stl")
     tool = TOOL.replace("shape = {{ sphere = 0.02 }}", 'mesh = "box.stl"\nunits = "m"\ndeviation_mm = 2')
-    more = 'mass = 4\ncom_tolerance = 0.02\n[[safety]]\nkind = "effective_mass"\nat = "arm"\nlimit = 900'
+    more = f"mass = 4\n{EVEN}com_tolerance = 0.02\n"
+    more += '[[safety]]\nkind = "effective_mass"\nat = "arm"\nlimit = 900'
     text = FLOATING + TWO_R + tool.format(more)
     cell = made(tmp_path, text, {"arm.urdf": two_r(masses=(0.1, 0.1)), "box.stl": box})
     state = state_at(cell, arm=((0.2, 1.0), (1.0, -2.0)))

@@ -100,10 +100,6 @@ KINDS = {
     ),
     "polytope with a free moment": (TWO_R, POLYTOPE + 'definition = "free_moment"\n'),
     "box of torques": (TWO_R, POLYTOPE + 'definition = "torque_box"\n'),
-    "mass with tolerances": (
-        TWO_R + "mass_tolerance = 0.01\n",
-        'kind = "effective_mass"\nat = "arm"\nlimit = 60\nalong = "motion"\n',
-    ),
     "field that tilts": (TWO_R + TILTS, DEVICE + 'sensor = "mat"\n'),
 }
 

@@ -20,10 +20,10 @@ from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
 
 POSE = ((0.0, np.pi / 2), (1.0, -2.0))
-GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n{more}\n'
-PART = (
-    '[[workpieces]]\nname = "part"\non = "grip"\nshape = {{ box = [0.1, 0.2, 0.3] }}\nmass = {mass}\n{more}\n'
-)
+GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n'
+GRIP += "uniform_density = true\n{more}\n"
+PART = '[[workpieces]]\nname = "part"\non = "grip"\nshape = {{ box = [0.1, 0.2, 0.3] }}\nmass = {mass}\n'
+PART += "uniform_density = true\n{more}\n"
 PERSON = """[[humans]]
 name = "op"
 stature = 1.75
@@ -307,13 +307,20 @@ def test_a_centre_of_mass_that_is_off_in_any_direction_is_within_the_interval(tm
 
 def test_a_density_that_is_off_is_a_mass_that_is_off(tmp_path):
     """And a tolerance of a density that nobody gave is refused."""
-    text = FLOATING + TWO_R + GRIP.format(mass=0.7, more="MORE").replace("mass = 0.7\nMORE", "{}")
+    text = (
+        FLOATING
+        + TWO_R
+        + GRIP.format(mass=0.7, more="MORE").replace("mass = 0.7\nuniform_density = true\nMORE", "{}")
+    )
     text += criterion("kinetic_energy", 'robot = "arm"')
     density = 0.7 / (4 / 3 * np.pi * 0.02**3)
     by_density, by_mass = (
         results_at(made(tmp_path / str(i), text.replace("{}", more), {"arm.urdf": two_r()}), arm=POSE)["it"]
         for i, more in enumerate(
-            (f"density = {density}\ndensity_tolerance = 0.1", "mass = 0.7\nmass_tolerance = 0.1")
+            (
+                f"density = {density}\ndensity_tolerance = 0.1",
+                "mass = 0.7\nuniform_density = true\nmass_tolerance = 0.1",
+            )
         )
     )
     assert by_density.interval == pytest.approx(by_mass.interval, rel=1e-9)
@@ -423,12 +430,14 @@ def test_torques_that_a_model_needs_are_not_within_where_masses_may_be_off(tmp_p
         judge(state)
         return judge(engine.tick())[0]
 
-    sure = said("sure", "")
+    even = "uniform_density = true\n"
+    sure = said("sure", even)
     assert sure.verdict == "within", sure.reason
-    off = said("off", "mass_tolerance = 0.4\n")
+    off = said("off", f"{even}mass_tolerance = 0.4\n")
     assert off.verdict == "undecided"
     assert "mass_tolerance of grip ± 40 % not followed in torques that the model needs" in off.reason
-    # A centre says that density is not uniform; moments of inertia do not count for what stands.
+    assert said("alone", "").verdict == "undecided"
+    # A centre alone says nothing of moments; these do not count for what stands.
     off = said("turned", "com = [0.03, 0, 0]\n")
     assert off.verdict == ("within" if kind == "force_polytope" else "undecided")
     given = "com = [0.03, 0, 0]\ninertia = [0.01, 0.01, 0.01, 0, 0, 0]\n"

@@ -40,6 +40,8 @@ class Quantity:
     """Relative uncertainty, of an estimate that has a bound; 0 when stated."""
     spread_error: float = 0.0
     """Of a mass: `Inertial.spread_error`."""
+    within: float = 0.0
+    """Of a mass: `Inertial.within` [m]."""
     gyration: float = 0.0
     """Of a mass: `Inertial.gyration` [m]."""
 

@@ -87,13 +87,18 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
         for link in mechanism.description.links
         if link.inertial is not None and link.inertial.gyration
     ]
-    things = (model.bodies[index] for index in mechanism.carried)
-    turned += [body.owner for body in things if body.mass is not None and body.mass.gyration]
+    weighed = [model.bodies[index] for index in mechanism.carried if model.bodies[index].mass is not None]
+    turned += [body.owner for body in weighed if body.mass is not None and body.mass.gyration]
     found += [
         Input(
             name=f"moments of inertia of {name}", value="any that fit into its shape", origin=Origin.MISSING
         )
         for name in turned
+    ]
+    found += [
+        Input(name=f"where the mass of {body.owner} is", value="anywhere in its shape", origin=Origin.MISSING)
+        for body in weighed
+        if body.mass is not None and body.mass.within
     ]
     found += [
         Input(name=text.removeprefix("nobody gave ").strip(), origin=Origin.MISSING)

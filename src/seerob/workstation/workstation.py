@@ -193,11 +193,18 @@ class Body(_Table, frozen=True, kw_only=True):
     mass: Mass
     """Mass [kg]."""
     com: Metres3 | None = None
-    """Centre of mass in the link's frame [m]; from the shape at uniform density when not given."""
+    """Centre of mass in the link's frame [m]; anywhere in the hull of its shape when not given."""
     inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
-    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; any that fit into its shape when not
+    given."""
+    uniform_density: bool = False
+    """Whether the link is of one density throughout, so that `com` and `inertia` follow from its shape."""
     source: str = "workstation file"
     """Where the figures are from, for the report."""
+
+    def __post_init__(self) -> None:
+        if self.uniform_density and self.inertia is not None:
+            raise ValueError("inertia is given, and follows from uniform_density: keep one")
 
 
 class Thing(_Table, frozen=True, kw_only=True):
@@ -237,11 +244,15 @@ class Thing(_Table, frozen=True, kw_only=True):
     mass: Mass | None = None
     """Mass [kg]; by `density` when not given, and with neither nobody knows it."""
     com: Metres3 | None = None
-    """Centre of mass in its own frame [m]."""
+    """Centre of mass in its own frame [m]; of a `mass`, anywhere in the hull of its shape when not given."""
     inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
-    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]."""
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; of a `mass`, any that fit into its shape
+    when not given."""
     density: Density | None = None
     """Uniform density [kg/m³] to compute the mass from the shape."""
+    uniform_density: bool = False
+    """Whether a `mass` is of one density throughout, as of a block of steel that was weighed, so that `com`
+    and `inertia` follow from the shape; a gripper with a motor is not."""
     color: tuple[Share, Share, Share] | None = None
     """Red, green, blue in 0…1."""
 
@@ -272,6 +283,8 @@ class Thing(_Table, frozen=True, kw_only=True):
             raise ValueError("inertia needs mass and com beside it")
         if self.com is not None and self.mass is None:
             raise ValueError("com needs mass beside it")
+        if self.uniform_density and (self.mass is None or self.inertia is not None):
+            raise ValueError("uniform_density is of a mass without inertia: leave it out")
 
 
 class Mounted(Thing, frozen=True, kw_only=True):
@@ -284,7 +297,8 @@ class Mounted(Thing, frozen=True, kw_only=True):
     density_tolerance: Tolerance | None = None
     """How far its ``density`` may be off, as a share, and with it its mass."""
     com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
-    """How far its centre of mass may be from where it is, in any direction [m]."""
+    """How far its centre of mass may be from where it is, in any direction [m]; without `com`, from where
+    uniform density has it."""
     real: bool = False
     """Whether it exists where the twin is shown over the real cell (AR, a camera's picture): it is not drawn
     there, hides what is behind it, and counts in every figure as before."""

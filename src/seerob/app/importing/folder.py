@@ -280,13 +280,13 @@ def _robot(moving: Moving, name: str, files: dict[str, bytes]) -> dict[str, Any]
 def _stated_mass(inertial: Inertial) -> dict[str, Any]:
     """Mass properties as a workstation file has them, with what is known of how far they are off.
 
-    Where it is not known how the mass is spread, that follows from the shape again, as far as it tells it.
+    Where a shape tells centre and moments within bounds alone, they follow from it again.
     """
     values: dict[str, Any] = {"mass": _number(inertial.mass, 12)}
     if inertial.error > INTEGRATED:
         values["mass_tolerance"] = _share(inertial.error)
     if inertial.spread_error > inertial.error + INTEGRATED:
-        return values
+        return values | {"uniform_density": True}
     i = np.where(np.abs(inertial.inertia) > 1e-12 * np.trace(inertial.inertia), inertial.inertia, 0.0)
     six = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
     return values | {

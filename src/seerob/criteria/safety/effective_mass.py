@@ -261,7 +261,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return _Masses if together else None
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
-        r"""Least margin in a span; None of what moves something else too, and of tolerances of masses.
+        r"""Least margin in a span; None of what moves something else too.
+
+        Of tolerances of masses only along the motion: any rates x bound the mass, by the heaviest matrix.
 
         :math:`m_u = \min_x x^T M x` over joint rates with :math:`u^T J x = 1`, at one end of the span by
         :math:`x^* = m_u M^{-1} J^T u`. Elsewhere in the span these rates are no longer the best, so
@@ -284,7 +286,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """
         limit, frame = self.limit, model.frame(self.at)
         robot = model.carrier(frame)
-        if limit is None or not robot.alone or len(MassTolerances(model, robot)):
+        tolerances = MassTolerances(model, robot)
+        moves = self.toward is None and self.along == "motion"
+        if limit is None or not robot.alone or (len(tolerances) and not moves):
             return None
         if any(body.holder for body in model.bodies):
             return None
@@ -293,8 +297,10 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         local = frame.body_from_frame[:3, :3] @ offset + frame.body_from_frame[:3, 3]
         point = points.add(frame.mj, local)
         heavy = [int(b) for b in robot.mj_bodies if mj.body_mass[b] > 0]
+        most = np.array([tolerances.heaviest(body) for body in heavy]).reshape(-1, 2)
         masses = mj.body_mass[heavy]
-        radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / masses)
+        radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / masses) + most[:, 1]
+        masses = most[:, 0] * masses
         rows = [points.add(b, mj.body_ipos[b], r) for b, r in zip(heavy, radii.tolist(), strict=True)]
         data = mujoco.MjData(mj)
 
@@ -313,7 +319,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             noise = float((np.linalg.norm(J, axis=0) + changes) @ span.joint_noise[own])
             if not np.isfinite(changes).all():
                 return -math.inf
-            if self.toward is None and self.along == "motion" and span.fast[point] + noise <= STANDSTILL:
+            if moves and span.fast[point] + noise <= STANDSTILL:
                 return math.inf
             of_masses = span.T * np.array([points.column_changes(row, span, coupling) for row in rows])
             inverse = np.linalg.inv(M)
@@ -322,10 +328,12 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 """How much more the masses move by some rates, and the point less."""
                 return math.sqrt(masses @ (of_masses @ rates) ** 2), float(changes @ rates)
 
-            if self.toward is None and self.along == "motion":
+            if moves:
                 before, after = (velocity(*span.path.at(t)) for t in (span.begin, span.end))
                 u, turned = _turned(before, after, float(span.bend[point]) + noise)
                 pushed = inverse @ J.T @ u
+                if len(tolerances):
+                    M = tolerances.matrices(state, pushed).at((1,) * len(tolerances))
                 if (along := float(u @ J @ pushed)) > 0:
                     x = pushed / along
                     more, less = grown(np.abs(x))

@@ -13,9 +13,8 @@ from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.domains import at_least
-from seerob.core.errors import Undecided
 from seerob.core.snapshot import Basis, Result, Sphere
-from seerob.core.tolerances import Spread, deciding, spread
+from seerob.core.tolerances import Shifts, Spread, deciding, spread
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion
@@ -84,8 +83,8 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         aboard = _aboard(model, robot)
         for each in (robot, *aboard):
             each.require_masses(self.name)
-        masses, alone = MassTolerances(model, robot), robot.alone and not aboard
-        off_aboard = next((each.name for each in aboard if len(MassTolerances(model, each))), "")
+        alone = robot.alone and not aboard
+        masses = tuple(MassTolerances(model, each) for each in (robot, *aboard))
         beside = (*robot.riders, *(each.name for each in aboard))
         others = tuple(dict.fromkeys((*model.carriers_of(robot.name), *beside)))
 
@@ -97,23 +96,15 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             else:
                 energy = sum(energy_of(cast("State", twin), each) for each in (robot, *aboard))
             low = high = energy
-            if off_aboard:
-                raise Undecided(
-                    f"{off_aboard}: how far its masses may be off is not followed on what moves it"
-                )
-            if len(masses):
-                if not masses.own:
-                    raise Undecided(
-                        f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
-                    )
+            if any(map(len, masses)):
                 ends = self._ends(masses, cast("State", twin), energy)
                 low, high = ends.low, ends.high
             error = twin.speed_error(robot)
             if error is not None:
                 # √(2E) is a norm of the velocities: it is off by no more than that of their errors.
                 M = twin.mass_matrix(robot)
-                if len(masses):
-                    M = masses.matrices(cast("State", twin)).at((1,) * len(masses))
+                if len(masses[0]):
+                    M = masses[0].matrices(cast("State", twin)).at((1,) * len(masses[0]))
                 off = np.sqrt(np.einsum("...ii,...i->...", M, error**2))
                 low = 0.5 * np.maximum(np.sqrt(2 * np.maximum(low, 0.0)) - off, 0.0) ** 2
                 high = 0.5 * (np.sqrt(2 * np.maximum(high, 0.0)) + off) ** 2
@@ -123,22 +114,34 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return compute
 
     @staticmethod
-    def _ends(masses: MassTolerances, state: State, energy: float | Array) -> Spread:
-        """Of the energy: what may be off moves by the robot's own joints, whatever else has energy, too."""
-        matrices, qd = masses.matrices(state), state.qd(masses.robot)
-        beside = energy - kinetic_energy(matrices.M, qd)
-        return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd) + beside, len(masses))
+    def _ends(masses: tuple[MassTolerances, ...], state: State, energy: float | Array) -> Spread:
+        """Of the energy: by the mass matrix where its own joints move all, else by each body's motion."""
+        first = masses[0]
+        if len(masses) == 1 and first.own:
+            matrices, qd = first.matrices(state), state.qd(first.robot)
+            beside = energy - kinetic_energy(matrices.M, qd)
+            return spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd) + beside, len(first))
+        more = [(len(each), each.energies(state)) for each in masses]
+
+        def shifted(shifts: Shifts) -> Array:
+            found, begin = np.asarray(energy, float), 0
+            for count, each in more:
+                found, begin = found + each(shifts[begin : begin + count]), begin + count
+            return np.asarray(np.maximum(found, 0.0))
+
+        return spread(shifted, sum(map(len, masses)))
 
     def present(self, model: Model) -> Present:
         """Return the function that draws a sphere at the tool's working point."""
         robot = model.mover(self.robot)
-        masses = MassTolerances(model, robot)
+        masses = tuple(MassTolerances(model, each) for each in (robot, *_aboard(model, robot)))
+        tolerances = [tolerance for each in masses for tolerance in each.tolerances]
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
             place, energy, reason = state.drawn_point(robot.tip, ORIGIN), figure.number, ""
             if verdict is Verdict.UNDECIDED:
-                widths = self._ends(masses, state, energy).widths if len(masses) else np.zeros(0)
-                reason = deciding(masses.tolerances, widths) or NOISE
+                widths = self._ends(masses, state, energy).widths if tolerances else np.zeros(0)
+                reason = deciding(tolerances, widths) or NOISE
 
             return Shown(reason, partial(_sphere, self, place, energy, verdict))
 
@@ -168,13 +171,18 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         robot = model.mover(self.robot)
         if self.limit is None:
             return None
-        tolerances = MassTolerances(model, robot)
         every = (robot, *_aboard(model, robot))
+        tolerances = [MassTolerances(model, each) for each in every]
         bodies = [int(b) for each in every for b in each.mj_bodies]
         dofs = np.concatenate([each.v_address for each in every])
-        limit, changes = self.limit, change_of_motion(model, bodies, dofs, points, tolerances.heaviest)
+
+        def most_of(body: int) -> tuple[float, float]:
+            factors, ways = zip(*(each.heaviest(body) for each in tolerances), strict=True)
+            return max(factors), max(ways)
+
+        limit, changes = self.limit, change_of_motion(model, bodies, dofs, points, most_of)
         mj, data, full = model.mj, mujoco.MjData(model.mj), np.zeros((model.mj.nv, model.mj.nv))
-        heaviest = np.array([tolerances.heaviest(body) for body in bodies]).reshape(-1, 2)
+        heaviest = np.array([most_of(body) for body in bodies]).reshape(-1, 2)
         total = math.sqrt(float(heaviest[:, 0] @ mj.body_mass[bodies]))
 
         def noise(span: Span) -> float:

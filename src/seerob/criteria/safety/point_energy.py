@@ -3,7 +3,7 @@ r"""Kinetic energy of a robot at a point of it: that of its effective mass there
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 from msgspec import Meta
@@ -13,13 +13,14 @@ from seerob.core.domains import at_least
 from seerob.core.errors import Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Basis, Sphere
+from seerob.core.tolerances import Shifts, Spread, deciding, spread
 from seerob.core.transforms import Array
 from seerob.core.verdict import Verdict
 from seerob.criteria.criterion import Criterion, Lowest
 from seerob.criteria.figure import Compute, Figure, Present, Shown, Twin
 from seerob.criteria.noisy_speeds import NOISE
 from seerob.model import provenance
-from seerob.model.model import Model
+from seerob.model.model import Frame, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.moving_base import velocity_of
 from seerob.twin.spans import Points, Span, change_of_motion
@@ -78,31 +79,54 @@ class PointEnergy(Criterion, frozen=True, kw_only=True):
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         robot.require_masses(self.name)
-        offset, toleranced = np.array(self.offset), len(MassTolerances(model, robot))
+        offset, masses = np.array(self.offset), MassTolerances(model, robot)
 
         def compute(twin: Twin) -> Figure:
-            if toleranced or not robot.alone:
-                what = "mass_tolerance is" if toleranced else "what carries it or rides on it is"
-                raise Undecided(f"{robot.name}: {what} not followed here: take kinetic_energy")
+            if not robot.alone:
+                raise Undecided(
+                    f"{robot.name}: what carries it or rides on it is not followed here: take kinetic_energy"
+                )
             velocity = velocity_of(twin, frame, robot, offset)[..., :3]
             energy = point_energy(twin.inverse_effective_mass(frame, robot, offset), velocity)
-            return Figure(energy if twin.many else float(energy), self.limit)
+            if not len(masses):
+                return Figure(energy if twin.many else float(energy), self.limit)
+            ends = self._ends(masses, cast("State", twin), frame, velocity)
+            return Figure(float(energy), self.limit, (ends.low, ends.high))
 
         return compute
+
+    def _ends(self, masses: MassTolerances, state: State, frame: Frame, velocity: Array) -> Spread:
+        """Of the energy: the velocity is that of the joints, whatever they move weighs."""
+        J_v = state.jacobian(frame, masses.robot, np.array(self.offset))[:3]
+        pushed = np.asarray(np.linalg.solve(state.mass_matrix(masses.robot), J_v.T @ velocity), float)
+        matrices = masses.matrices(state, pushed)
+
+        def at(shifts: Shifts) -> Array:
+            return point_energy(J_v @ np.linalg.solve(matrices.at(shifts), J_v.T), velocity)
+
+        return spread(at, len(masses))
 
     def present(self, model: Model) -> Present:
         """Return the function that draws a sphere at the point."""
         frame, offset = model.frame(self.at), np.array(self.offset)
+        robot = model.carrier(frame)
+        masses = MassTolerances(model, robot)
 
         def present(state: State, figure: Figure, verdict: Verdict | None) -> Shown:
-            place, energy = state.drawn_point(frame, offset), figure.number
+            place, energy, reason = state.drawn_point(frame, offset), figure.number, ""
 
             def draw() -> tuple[Sphere, ...]:
                 label = figures.worded(energy, self.limit, self.unit, at_most=True)
                 radius = DRAWN * max(energy, 0.0) ** (1 / 3)
                 return (Sphere(center=tuple(place().tolist()), radius=radius, label=label, verdict=verdict),)
 
-            return Shown(NOISE if verdict is Verdict.UNDECIDED else "", draw)
+            if verdict is Verdict.UNDECIDED:
+                widths = np.zeros(0)
+                if len(masses):
+                    velocity = velocity_of(state, frame, robot, offset)[:3]
+                    widths = self._ends(masses, state, frame, velocity).widths
+                reason = deciding(masses.tolerances, widths) or NOISE
+            return Shown(reason, draw)
 
         return present
 
@@ -117,20 +141,23 @@ class PointEnergy(Criterion, frozen=True, kw_only=True):
         r"""Least margin in a span, by the energy of the whole robot, which is never less than at a point.
 
         :math:`\sqrt{2E}` of the whole is a norm of its velocities, and changes by no more than the norm of
-        how much these do (`seerob.twin.spans.change_of_motion`).
+        how much these do (`seerob.twin.spans.change_of_motion`), with the heaviest masses there may be.
         """
         robot, limit = model.carrier(model.frame(self.at)), self.limit
-        if limit is None or not robot.alone or len(MassTolerances(model, robot)):
+        if limit is None or not robot.alone:
             return None
-        changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points)
+        masses = MassTolerances(model, robot)
+        changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points, masses.heaviest)
         dofs = robot.v_address
 
         def lowest(state: State, span: Span) -> float:
             change, _ = changes(span)
             if not math.isfinite(change) or span.joint_noise[dofs].any():
                 return -math.inf
-            qd = state.qd(robot)
-            whole = math.sqrt(max(float(qd @ state.mass_matrix(robot) @ qd), 0.0))
+            qd, M = state.qd(robot), state.mass_matrix(robot)
+            if len(masses):
+                M = masses.matrices(state).at((1,) * len(masses))
+            whole = math.sqrt(max(float(qd @ M @ qd), 0.0))
             return limit - 0.5 * (whole + change) ** 2
 
         return lowest

@@ -490,7 +490,7 @@ class Contacts:
         invalid_reason = ""
         if mover is not None:
             k, F_d = self.arrays.stiffness * (1 - spec.stiffness_tolerance), spec.drive_force
-            if len(self.ends.masses):
+            if self.ends.masses.weighs_otherwise:
                 invalid_reason = (
                     f"mass_tolerance is not followed on what moves {robot.name}: leave it out here"
                 )
@@ -518,7 +518,7 @@ class Contacts:
         )  # fmt: skip
 
     def lowest(self, points: Points) -> Lowest | None:
-        r"""Least margin in a span, a share of what is permitted; none of tolerances, carriers, measurements.
+        r"""Least margin in a span, a share of what is permitted; none of carriers and measurements.
 
         Surfaces are as fast as they get in the span, hit whatever they may come near and clamp whatever they
         may clamp. Of the effective mass along the motion, :math:`m_u v^2 \le 2E`, E the kinetic energy of
@@ -526,16 +526,19 @@ class Contacts:
         """
         spec, model, robot = self.spec, self.model, self.robot
         held = any(body.holder for body in model.bodies)
-        if not self.moving or not robot.alone or self.behind.pushed or self.ends.tolerances or held:
+        if not self.moving or not robot.alone or self.behind.pushed or held:
             return None
         if spec.measurements is not None:
             return None
         moving = rows_of(self.moving)
         reach = np.array([model.bodies[i].radius + model.bodies[i].deviation for i in self.moving])
-        changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points)
-        excluded = self.excluded
+        masses = self.ends.masses
+        if len(self.ends.tolerances) > len(masses):
+            return None
+        changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points, masses.heaviest)
+        excluded, heaviest = self.excluded, (1,) * len(masses)
         limited = np.isin(np.arange(len(REGIONS)), self.in_regions)
-        simplified = self.behind.simplified(None)
+        simplified = masses.simplified(self.behind.simplified(None), heaviest)
 
         def turned(span: Span) -> Array:
             """How much faster surfaces are than the points whose direction counts [m/s], shape (b,)."""
@@ -547,6 +550,8 @@ class Contacts:
         def energy(state: State, span: Span) -> float:
             qd = state.qd(robot)
             M, off = state.mass_matrix(robot), span.joint_noise[robot.v_address[robot.own]]
+            if heaviest:
+                M = masses.matrices(state).at(heaviest)
             now = math.sqrt(float(qd @ M @ qd)) + math.sqrt(float(np.diagonal(M) @ off**2))
             return (now + changes(span)[0]) ** 2 / 2
 

@@ -586,10 +586,12 @@ def _inertial(
         return None, "inertial without a mass", None
     kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
     # As an import of ours writes them, of a mass by density.
-    told = "error", "spread_error", "gyration"
+    told = "error", "spread_error", "within", "gyration"
     off = [float(reader.numbers(mass, key_, f"{key}.mass", (0.0,))[0]) for key_ in told]
     if not all(0 <= share <= 1e3 for share in off):
-        reader.problem(f"{key}.mass.error", f"is {off}", "a share from 0 up, of gyration a length in m")
+        reader.problem(
+            f"{key}.mass.error", f"is {off}", "a share from 0 up, of within and gyration a length in m"
+        )
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
@@ -608,7 +610,8 @@ def _inertial(
         source=f"{reader.file}: link {name}",
         error=off[0],
         spread_error=off[1],
-        gyration=off[2],
+        within=off[2],
+        gyration=off[3],
     )
     kept, level, text = lint.plausible_inertial(made, body=body)
     if text:

@@ -165,6 +165,7 @@ def _inertial(link: Element, inertial: Inertial, *, plain: bool) -> None:
     off = {
         "error": inertial.error,
         "spread_error": inertial.spread_error,
+        "within": inertial.within,
         "gyration": inertial.gyration,
     }
     said = {} if plain else {key: repr(float(one)) for key, one in off.items() if one > 0}

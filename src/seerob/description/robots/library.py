@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -31,7 +31,7 @@ from seerob.core.transforms import Array
 from seerob.description import lint
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
 from seerob.description.robots import library_names
-from seerob.description.shapes import moments, shapes
+from seerob.description.shapes import mass_properties, moments, shapes
 
 NOTE = "envelope made by seerob, not the maker's mesh"
 
@@ -235,7 +235,7 @@ def _inertial(entry: Table, block: Table, solids: Sequence[Solid]) -> Inertial:
         known = moments.combined(map(moments.of_solid, solids))
         found = known.inertial(mass=float(mass), origin=origin, source=source, error=error)
         corners = np.vstack([solid.mesh.vertices for solid in solids if solid.mesh is not None])
-        return replace(found, within=float(np.linalg.norm(corners - found.com, axis=1).max()))
+        return mass_properties.anywhere(found, corners, 0.0)
     xx, yy, zz, xy, xz, yz = entry["inertia"]
     return Inertial(
         mass=float(mass),

@@ -188,6 +188,7 @@ def _overlap(corners: Array, centers: Array) -> NDArray[np.bool_]:
 __all__ = [
     "Moments",
     "about_its_centre",
+    "anywhere",
     "boxes_meet",
     "combined",
     "from_shape",
@@ -206,7 +207,10 @@ PATCHED = 0.2
 
 
 OFF_CENTRE = 1e-3
-"""How far a given centre of mass may be from that of uniform density without a finding [m]: a choice."""
+"""How far a centre of mass that is given may be from that of uniform density, where that is said [m]: a
+choice."""
+LEAST_GYRATION = 1e-3
+"""Radius of gyration that is counted at least of what may be spread anyhow [m]: a choice."""
 SLITS = 1e-9
 """Share of the surface that is none: edges of unequal length that meet leave holes without an area."""
 
@@ -310,46 +314,47 @@ def from_shape(
     return inertial, tuple(findings)
 
 
-def about_its_centre(
-    uniform: Inertial, com: Sequence[float], box: tuple[Array, Array], *, subject: str
-) -> tuple[Inertial, tuple[Finding, ...]]:
-    """Mass properties of what has its centre of mass elsewhere than uniform density has it.
+def anywhere(uniform: Inertial, points: Array, beyond: float) -> Inertial:
+    """Mass properties of what may be spread anyhow within its shape; told as those of uniform density.
 
-    Its moments are told as those of uniform density, and may be any that a body in that box can have. Where
-    the box does not hold the centre, nothing that depends on the body is within.
+    Args:
+        uniform: At uniform density.
+        points: Their convex hull, dilated by ``beyond`` [m], holds all of it, shape (n, 3) [m].
+        beyond: How far.
+    """
+    far = float(np.linalg.norm(points - uniform.com, axis=1).max()) + beyond
+    # Of a mass that is given, there is nothing else that its shape leaves open.
+    return replace(uniform, within=far, spread_error=0.0 if uniform.error == 0.0 else uniform.spread_error)
+
+
+def about_its_centre(
+    uniform: Inertial, com: Sequence[float], points: Array, beyond: float, *, off: float = 0.0
+) -> Inertial:
+    """Mass properties of what has a known centre of mass and may be spread anyhow about it.
+
+    Its moments are told as those of uniform density, and may be any that a body has that lies in the box and
+    in the ball about its shape. In a ball of radius δ, the mean square distance from a centre that is d from
+    the ball's is no more than δ² − d².
 
     Args:
         uniform: At uniform density.
         com: The centre of mass [m].
-        box: Lowest and highest corner of one that holds all of it [m].
-        subject: Full name of the body: its own, or that of its robot and a link's.
+        points: Their convex hull, dilated by ``beyond`` [m], holds all of it, shape (n, 3) [m].
+        beyond: How far.
+        off: How far its centre may be from there, in any direction [m].
     """
     inertial = replace(uniform, com=np.array(com, float))
-    off = float(np.linalg.norm(inertial.com - uniform.com))
-    if off <= OFF_CENTRE:
-        return inertial, ()
-    outside = np.linalg.norm(np.maximum(np.maximum(box[0] - com, com - box[1]), 0.0))
-    if outside > 1e-9:
-        text = (
-            f"its centre of mass is {1e3 * outside:.3g} mm outside the box around its shape, and how mass is "
-            "spread that no shape shows, nobody knows: give inertia"
-        )
-        return inertial, (
-            Finding(level="warning", subject=subject, text=text, holds=(subject.partition("/")[0],)),
-        )
-    gyration = max(mass_bounds.largest_gyration(inertial.com, *box), OFF_CENTRE)
+    reach = beyond + off
+    box = points.min(axis=0) - reach, points.max(axis=0) + reach
+    far = anywhere(uniform, points, beyond).within
+    away = max(float(np.linalg.norm(inertial.com - uniform.com)) - off, 0.0)
+    in_ball = math.sqrt(max(far**2 - away**2, 0.0))
+    gyration = max(min(mass_bounds.largest_gyration(inertial.com, *box), in_ball), LEAST_GYRATION)
     # Those of uniform density may be more than any that has its centre there.
     share = min(1.0, inertial.mass * gyration**2 / float(np.linalg.eigvalsh(inertial.inertia)[-1]))
     inertial = replace(inertial, gyration=gyration, inertia=share * inertial.inertia)
-    if uniform.error == 0.0:
-        # Mass and centre are given, and the moments have a bound of their own.
-        inertial = replace(inertial, spread_error=0.0)
-    text = (
-        f"moments of inertia are those of uniform density, and its centre of mass is {1e3 * off:.3g} mm from "
-        "where uniform density has it: give inertia, or what rests on them has an interval of any that fit "
-        "into its shape"
-    )
-    return inertial, (Finding(level="assumed", subject=subject, text=text),)
+    # Where mass and centre are given, the moments have a bound of their own.
+    return replace(inertial, spread_error=0.0) if uniform.error == 0.0 else inertial
 
 
 def _of_given(mesh: Mesh, around: float, moments: Moments, error: float, everything: float) -> float:

@@ -19,7 +19,6 @@ from seerob.core.errors import UnknownName
 from seerob.core.shapes import Mesh, Solid
 from seerob.core.snapshot import Finding, Origin
 from seerob.core.transforms import Array, rotation_from_rpy, transform
-from seerob.description import lint
 from seerob.description.description import Inertial
 from seerob.description.robots.library import NOTE, shapes_for
 from seerob.description.shapes import mass_properties
@@ -34,7 +33,7 @@ class LibraryTool:
     solids: tuple[Solid, ...]
     visual: tuple[Mesh, ...]
     inertial: Inertial | None
-    """None where no mass is published; where a mass alone is, spread over the envelope."""
+    """None where no mass is published; where a mass alone is, anywhere in the envelope."""
     tcp: Array | None
     """Its working point, shape (4, 4) [m]; None where no source says one."""
     findings: tuple[Finding, ...]
@@ -82,12 +81,14 @@ def _inertial(table: dict[str, Any], solids: tuple[Solid, ...], tool: str) -> In
     origin, source, mass = Origin(table["origin"]), table["source"], float(table["mass"])
     meshes = [solid.mesh for solid in solids if solid.mesh is not None]
     spread, _ = mass_properties.from_shape(meshes, mass=mass, subject=tool)
-    com = table.get("com", spread.com)
     if "inertia" in table:
         xx, yy, zz, xy, xz, yz = table["inertia"]
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
-        return Inertial(mass, np.array(com, float), inertia, origin, source)
-    source = f"{source}; spread over the envelope"
-    # Who gives a mass instead is not told of these moments: a file says itself that its source has none.
-    inertial, _ = mass_properties.about_its_centre(spread, com, lint.box(solids), subject=tool)
-    return replace(inertial, origin=origin, source=source)
+        return Inertial(mass, np.array(table["com"], float), inertia, origin, source)
+    # Who gives a mass instead is not told of these: a file says itself what its source has not.
+    points = np.vstack([mesh.vertices for mesh in meshes])
+    if "com" in table:
+        inertial = mass_properties.about_its_centre(spread, table["com"], points, 0.0)
+    else:
+        inertial = mass_properties.anywhere(spread, points, 0.0)
+    return replace(inertial, origin=origin, source=f"{source}; anyhow in the envelope")

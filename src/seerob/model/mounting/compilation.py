@@ -584,6 +584,7 @@ def _weight(inertial: Inertial) -> Quantity:
         inertial.source,
         inertial.error,
         inertial.spread_error,
+        inertial.within,
         inertial.gyration,
     )
 

@@ -23,7 +23,7 @@ from seerob.description.shapes.mesh_bodies import is_closed, joined
 from seerob.description.shapes.mesh_mending import enclosing
 from seerob.description.shapes.moments import signed_volume
 from seerob.description.tools import library
-from seerob.model.mounting.specification import Mounting, pose_matrix
+from seerob.model.mounting.specification import Mounting, extreme_points, pose_matrix
 from seerob.workstation.tables.sensors import Sensor
 from seerob.workstation.workstation import Area, Mounted, Shape, Thing
 from seerob.workstation.workstation import Body as BodyTable
@@ -38,6 +38,8 @@ CYLINDER_SIDES = 96
 NO_DEPTH = (
     "its mesh has holes, and nobody says how far beyond their rims its surface may lie: give hole_depth"
 )
+ROUNDING = 1e-9
+"""Outside of a box by no more than this is none [m]."""
 VISIBLE = 1e-4
 """How far what is shown may be off without a finding [m]."""
 
@@ -148,7 +150,7 @@ def load_thing(
     inertial: Inertial | None = None
     more: tuple[Finding, ...] = ()
     if needs_mass and (thing.mass is not None or thing.density is not None):
-        inertial, more = _inertial(thing, whole, solids, off, source)
+        inertial, more = _inertial(thing, whole, solids, off, source, file)
     elif needs_mass and known is not None:
         inertial = known.inertial
     elif thing.mass is not None and thing.com is not None:
@@ -234,21 +236,25 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
 
 
 def _inertial(
-    thing: Thing, meshes: list[Mesh], solids: Sequence[Solid], deviation: float, source: str
+    thing: Thing, meshes: list[Mesh], solids: Sequence[Solid], deviation: float, source: str, file: str
 ) -> tuple[Inertial | None, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
         return given_inertial(thing.mass, thing.com, thing.inertia, "workstation file"), ()
     inertial, findings = _spread(thing, meshes, deviation)
     if np.isinf(inertial.spread_error):
         return None, findings
-    if thing.com is not None:
-        beyond = thing.hole_depth or 0.0
-        if isinstance(thing, Mounted):
-            beyond += thing.com_tolerance or 0.0
-        inertial, uneven = mass_properties.about_its_centre(
-            inertial, thing.com, _box(solids, beyond), subject=thing.name
+    if thing.mass is not None:
+        off = (thing.com_tolerance or 0.0) if isinstance(thing, Mounted) else 0.0
+        inertial, told = _as_spread(
+            inertial,
+            thing,
+            solids,
+            off=off,
+            beyond=thing.hole_depth or 0.0,
+            subject=thing.name,
+            where=(file, ""),
         )
-        findings += uneven
+        findings += told
     if thing.mass is not None:
         # The mass itself was given; only how it is spread follows from the shape.
         inertial = replace(inertial, origin=Origin.GIVEN, error=0.0, source=f"workstation file; {source}")
@@ -260,11 +266,66 @@ def _inertial(
     return inertial, findings
 
 
-def _box(solids: Sequence[Solid], beyond: float) -> tuple[Array, Array]:
-    """Lowest and highest corner [m] of the box that holds all of a body, farther out by what is not known."""
-    low, high = lint.box(solids)
-    margin = beyond + max(solid.deviation for solid in solids)
-    return low - margin, high + margin
+def _as_spread(
+    uniform: Inertial,
+    table: Thing | BodyTable,
+    solids: Sequence[Solid],
+    *,
+    off: float,
+    beyond: float,
+    subject: str,
+    where: tuple[str, str],
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties of a given mass, as far as somebody says how it is spread, and what is told of it.
+
+    Args:
+        uniform: At uniform density.
+        table: What the user gave, without centre or inertia.
+        solids: Its shape.
+        off: How far its centre may be from where it is, as the file says [m].
+        beyond: How far it may reach out of its shape at holes [m].
+        subject: Full name of the body.
+        where: The workstation file and the key of the table in it, for messages.
+
+    Raises:
+        InputError: Its centre of mass is said to be where no uniform density has it.
+    """
+    com = uniform.com if table.com is None else np.array(table.com, float)
+    if table.uniform_density:
+        way = float(np.linalg.norm(com - uniform.com))
+        if way > mass_properties.OFF_CENTRE + off:
+            file, key = where
+            what = (
+                f"is {1e3 * way:.3g} mm from where uniform density has it, {uniform.com.round(4).tolist()} m"
+            )
+            remedy = "leave out com or uniform_density"
+            raise InputError.at(file, f"{key}com", what, remedy)
+        return replace(uniform, com=com), ()
+    points, radius = extreme_points(solids)
+    margin = radius + beyond + max(solid.deviation for solid in solids)
+    if table.com is None and not (off and isinstance(table, Thing)):
+        inertial = mass_properties.anywhere(uniform, points, margin)
+        text = (
+            "nobody says where in its shape its mass is: give com and inertia, or uniform_density = true "
+            "where that is so; what rests on them has an interval of all that fit into its shape"
+        )
+    else:
+        reach = margin + off
+        beside = np.maximum(points.min(axis=0) - reach - com, com - points.max(axis=0) - reach)
+        if (outside := float(np.linalg.norm(np.maximum(beside, 0.0)))) > ROUNDING:
+            text = (
+                f"its centre of mass is {1e3 * outside:.3g} mm outside the box around its shape, and how "
+                "mass is spread that no shape shows, nobody knows: give inertia"
+            )
+            holds = (subject.partition("/")[0],)
+            found = Finding(level="warning", subject=subject, text=text, holds=holds)
+            return replace(uniform, com=com), (found,)
+        inertial = mass_properties.about_its_centre(uniform, com.tolist(), points, margin, off=off)
+        text = (
+            "nobody says how its mass is spread about its centre: give inertia; what rests on it has an "
+            "interval of all moments that fit into its shape"
+        )
+    return inertial, (Finding(level="assumed", subject=subject, text=text),)
 
 
 def _spread(thing: Thing, meshes: list[Mesh], deviation: float) -> tuple[Inertial, tuple[Finding, ...]]:
@@ -471,11 +532,16 @@ def overridden_link(
         inertial = given_inertial(table.mass, table.com, table.inertia, table.source)
     else:
         inertial, findings = spread()
-        if table.com is not None:
-            inertial, uneven = mass_properties.about_its_centre(
-                inertial, table.com, _box(link.solids, com_tolerance), subject=subject
-            )
-            findings += uneven
+        inertial, told = _as_spread(
+            inertial,
+            table,
+            link.solids,
+            off=com_tolerance,
+            beyond=0.0,
+            subject=subject,
+            where=(file, f"{key}."),
+        )
+        findings += told
         if table.inertia is not None:
             inertial = replace(inertial, inertia=symmetric(table.inertia))
         inertial = replace(inertial, source=f"{table.source}; rest from the shape")

@@ -66,6 +66,7 @@ class MassTolerances:
     def __init__(self, model: Model, robot: Mechanism) -> None:
         self._model, self.robot = model, robot
         names = {int(i): str(model.mj.body(int(i)).name) for i in robot.mj_bodies}
+        bodies = {name: i for i, name in names.items()}
         station = model.workstation
         found: list[_Off] = []
         for table in station.robots:
@@ -81,21 +82,23 @@ class MassTolerances:
                         (_estimated(link.inertial) for link in robot.description.links), default=0.0
                     ),
                 )
-                found += _of_links(robot, {name: i for i, name in names.items()}, table.mass_tolerance or 0.0)
+                found += _of_links(robot, bodies, table.mass_tolerance or 0.0)
                 if share := table.rotor_tolerance:
                     tolerance = Tolerance(f"rotor_tolerance of {table.name}", 100 * share, "%")
                     found.append(_Off(tolerance, (), share=share, rotors=True))
         for thing in (*station.tools, *station.workpieces):
-            bodies = [i for i, name in names.items() if name == thing.name or i in _held(model, thing)]
+            own_bodies = [i for i, name in names.items() if name == thing.name or i in _held(model, thing)]
             known = (body.mass for body in model.bodies if body.owner == thing.name)
             found += _offs(
                 thing.name,
-                bodies,
+                own_bodies,
                 mass=thing.mass_tolerance,
                 density=thing.density_tolerance,
                 com=thing.com_tolerance,
                 estimated=max(map(_estimated, known), default=0.0),
             )
+        if robot.role == "machine":
+            found += _of_links(robot, bodies, 0.0)
         found += _estimates(model, robot)
         self.tolerances = tuple(off.tolerance for off in found)
         self._offs = found
@@ -161,6 +164,11 @@ class MassTolerances:
         """What leaves centres of mass open, in words."""
         return tuple(str(off.tolerance) for off in self._offs if off.ways or off.spread)
 
+    @property
+    def weighs_otherwise(self) -> bool:
+        """Whether it may weigh more or less in all, wherever its masses are."""
+        return any(off.share or off.spread for off in self._offs if not off.rotors)
+
     def of_torques(self, *, at_rest: bool) -> tuple[str, ...]:
         """What leaves torques open, in words: moments of inertia do not where the robot stands."""
         return tuple(str(off.tolerance) for off in self._offs if not (at_rest and off.turned))
@@ -180,6 +188,27 @@ class MassTolerances:
         rates = state.qd(self.robot) if rates is None else rates
         parts = [off.parts(state, self.robot, rates) for off in self._offs]
         return Matrices(M, parts, lambda: self._without(state, M))
+
+    def energies(self, state: State) -> Callable[[Shifts], float]:
+        """How much more energy there is at shifted masses, whatever else moves what may be off [J].
+
+        Args:
+            state: The twin.
+
+        Raises:
+            Undecided: Not heard.
+        """
+        rates = state.data_of(self.robot.name, *self.robot.riders).qvel
+        parts = [off.parts(state, self.robot, rates, whole=True) for off in self._offs]
+        lost, gained = ([0.5 * float(rates @ part[k] @ rates) for part in parts] for k in (0, 2))
+
+        def more(shifts: Shifts) -> float:
+            return sum(
+                shift * (up if shift > 0 else down)
+                for shift, up, down in zip(shifts, gained, lost, strict=True)
+            )
+
+        return more
 
     def _without(self, state: State, M: Array) -> Array:
         """A mass matrix without all bodies that may be off by anything: no less is ever left of it."""
@@ -244,12 +273,12 @@ class _Off:
         """How far the mass of one of the bodies may be off [m]."""
         return self.ways[self.bodies.index(body)] if self.ways else 0.0
 
-    def parts(self, state: State, robot: Mechanism, qd: Array) -> _Bounds:
-        """What it makes of the mass matrix at its ends."""
-        n = len(robot.joints)
+    def parts(self, state: State, robot: Mechanism, qd: Array, *, whole: bool = False) -> _Bounds:
+        """What it makes of the mass matrix at its ends; of all that moves, when the whole is asked for."""
+        n = len(qd)
         found = [np.zeros((n, n)) for _ in range(3)]
         for body in self.bodies:
-            part = _Part.of(state, robot, body)
+            part = _Part.of(state, robot, body, whole=whole)
             way = self.way_of(body)
             share = max(self.share, self.spread)
             lost = min(share, 1.0) * part.matrix
@@ -259,7 +288,8 @@ class _Off:
             found = [a + b for a, b in zip(found, each, strict=True)]
         if self.rotors:
             spun = state.model.mj.dof_armature[robot.v_address]
-            matrix = self.share * robot.coupling.T @ (spun[:, None] * robot.coupling)
+            coupling = np.eye(n)[robot.v_address] if whole else robot.coupling
+            matrix = self.share * coupling.T @ (spun[:, None] * coupling)
             found = [a + matrix for a in found]
         lost, at_most, gained = found
         return _Bounds(lost, at_most, gained, self.anyhow or self.turned or self.spread >= 1)
@@ -276,12 +306,14 @@ class _Part:
     """In world axes (3, 3) [kg·m²]."""
 
     @classmethod
-    def of(cls, state: State, robot: Mechanism, body: int) -> _Part:
-        """Of a body of `mujoco`."""
+    def of(cls, state: State, robot: Mechanism, body: int, *, whole: bool = False) -> _Part:
+        """Of a body of `mujoco`; of the joints of all that moves, when the whole is asked for."""
         mj, data = state.model.mj, state.data_of(robot.name)
         linear, angular = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
         mujoco.mj_jacBodyCom(mj, data, linear, angular, body)
-        J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))
+        J_c, J_w = linear, angular
+        if not whole:
+            J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))
         turn = data.ximat[body].reshape(3, 3)
         return cls(float(mj.body_mass[body]), J_c, J_w, turn @ np.diag(mj.body_inertia[body]) @ turn.T)
 
@@ -373,15 +405,8 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
         off = tuple(body for body, of in known if (of.error, of.spread_error) == (share, spread))
         yield _off_by(f"masses of links of {robot.name}", off, share, spread, either)
     if anyhow := [(body, of) for body, of in known if of.within]:
-        widest, error = max(of.within for _, of in anyhow), max(of.error for _, of in anyhow)
-        yield _Off(
-            Tolerance(f"where masses are in links of {robot.name}", widest, "m"),
-            tuple(body for body, _ in anyhow),
-            ways=tuple(of.within for _, of in anyhow),
-            anyhow=True,
-            lighter=max(1 - error - either, 0.0),
-            heavier=(1 + error) * (1 + either),
-        )
+        name, error = f"where masses are in links of {robot.name}", max(of.error for _, of in anyhow)
+        yield _anywhere(name, {body: of.within for body, of in anyhow}, either, error)
     for body, of in known:
         if of.gyration:
             name = f"radius of gyration of {next(name for name, each in full.items() if each is of)}"
@@ -389,23 +414,47 @@ def _of_links(robot: Mechanism, bodies: Mapping[str, int], either: float) -> Ite
 
 
 def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
-    """Masses that follow from a density and a volume of which only bounds are known."""
+    """Masses of a density and a volume of which only bounds are known, and those that may be anywhere."""
     things = (*model.workstation.tools, *model.workstation.workpieces)
     given = {thing.name: thing for thing in things}
-    found = [(model.bodies[i], model.bodies[i].mj) for i in robot.carried]
+    # What has several pieces has its mass in the body that they are all fixed to.
+    of_name = {str(model.mj.body(int(i)).name): int(i) for i in robot.mj_bodies}
+    found = [(model.bodies[i], of_name.get(model.bodies[i].owner, model.bodies[i].mj)) for i in robot.carried]
     for thing in things:
         in_hand = _held(model, thing).intersection(robot.mj_bodies)
         found += [(body, i) for body in model.bodies if body.owner == thing.name for i in in_hand]
     for body, mj in found:
-        if body.mass is not None and _estimated(body.mass) > EXACT:
-            of = given.get(body.owner)
-            either = 0.0 if of is None else heavier_by_tolerances(of) - 1
+        if body.mass is None:
+            continue
+        of = given.get(body.owner)
+        either = 0.0 if of is None else heavier_by_tolerances(of) - 1
+        off = _estimated(body.mass)
+        if off > EXACT:
             yield _off_by(f"volume of {body.owner}", (mj,), body.mass.error, body.mass.spread_error, either)
-        if body.mass is not None and body.mass.gyration:
-            of = given.get(body.owner)
-            either = 0.0 if of is None else heavier_by_tolerances(of) - 1
-            name = f"radius of gyration of {body.owner}"
-            yield _turned(name, mj, body.mass.gyration, either, _estimated(body.mass))
+        if body.mass.gyration:
+            yield _turned(f"radius of gyration of {body.owner}", mj, body.mass.gyration, either, off)
+        if body.mass.within:
+            name = f"where the mass of {body.owner} is, of which nobody gave com and inertia,"
+            yield _anywhere(name, {mj: body.mass.within}, either, off)
+
+
+def _anywhere(name: str, within: Mapping[int, float], either: float, estimated: float) -> _Off:
+    """Masses that may be anywhere in balls about where they are told to be.
+
+    Args:
+        name: What is told as off.
+        within: Radii of these [m], by body of `mujoco`.
+        either: Share by which the masses may be off, as somebody says.
+        estimated: Share by which they are, as they are estimated.
+    """
+    return _Off(
+        Tolerance(name, max(within.values()), "m"),
+        tuple(within),
+        ways=tuple(within.values()),
+        anyhow=True,
+        lighter=max(1 - estimated - either, 0.0),
+        heavier=(1 + estimated) * (1 + either),
+    )
 
 
 def _turned(name: str, body: int, gyration: float, either: float, estimated: float) -> _Off:

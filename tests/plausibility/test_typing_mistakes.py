@@ -223,6 +223,16 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         "tools[0].tcp_outside",
         set(),
     ),
+    "a tool that stands out of the flange sideways": (
+        {"tool": CELL["tool"] + "\nat = { rpy_deg = [0, 90, 0] }\ntcp = { position = [0, 0, 0.1] }"},
+        "tools[0].across",
+        set(),
+    ),
+    "a gripper of the library on a flange whose x points out": (
+        {"tool": 'model = "library:onrobot_rg2"\nat = { rpy_deg = [0, -90, 0] }'},
+        "tools[0].across",
+        set(),
+    ),
     "metres in offset_mm": (
         {"limit": "limit = 1.0\noffset_mm = [0, 0, 0.13]"},
         "safety[0].offset",
@@ -638,7 +648,7 @@ def test_every_row_of_the_data_is_of_something() -> None:
         walk(TABLES[group], group)
         for what in FOLLOWS.get(group, ()):
             kinds |= {(f"{group}.{what}x" if what.endswith(".") else f"{group}.{what}", unit)
-                      for unit in ("m", "kg", "kg/m²", "kg/m³", "")}  # fmt: skip
+                      for unit in ("m", "rad", "kg", "kg/m²", "kg/m³", "")}  # fmt: skip
     walk(Engine, "engine")
     kinds.add(("engine.gravity.turned", "rad"))
     kinds.add(("safety.separation.stop.table.joints.share", ""))

@@ -18,8 +18,9 @@ from seerob.core.transforms import Array
 from seerob.description.lint import box
 from seerob.distance.depth import Depths
 from seerob.distance.least import Query
-from seerob.model.model import Body, Mechanism, Model
+from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting.chains import beyond_flange
+from seerob.model.mounting.specification import pose_matrix
 from seerob.workstation.plausibility.ranges import (
     Quantity,
     data,
@@ -43,6 +44,8 @@ LEVEL = 0.05
 """What is not farther from z = 0 stands there [m]."""
 TOUCHES = 0.01
 """A base that is so near to something stands on it, or beside it [m]."""
+ON_AXIS = 0.01
+"""A flange that is no farther from the axis of the last joint is on it [m]; a link that swings is not."""
 SIGHT = 50.0
 """Farther apart is not measured [m]."""
 
@@ -92,6 +95,7 @@ def _following(model: Model, place: _Home) -> Iterator[Quantity]:
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
     yield from _parts(model, place)
     yield from _misplaced(model, place)
+    yield from _across(model, place)
     yield from _bases(model, place)
     yield from _below(model, place)
     yield from _nobody(model, [place])
@@ -237,6 +241,35 @@ def _misplaced(model: Model, place: _Home) -> Iterator[Quantity]:
             )
 
 
+def _across(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How far tools point away from the axis of the last joint, where the flange is on it.
+
+    That is z of a tool of the library; of another one, on a robot of the library, the way from the flange to
+    its working point.
+    """
+    station = model.workstation
+    arms = {robot.name for robot in station.robots if robot.model.startswith("library:")}
+    carried = {tool.name for tool in station.tools}
+    for i, tool in enumerate(station.tools):
+        flange = None if tool.on in carried else model.frames.get(tool.on)
+        if flange is None or (axis := place.axis(model, flange)) is None:
+            continue
+        flange_from_tool, world_from_flange = pose_matrix(tool.at), place.pose(flange)
+        if tool.library is not None:
+            way, said = flange_from_tool[:3, 2], f"between the last joint's axis and z of {tool.name}"
+        elif tool.tcp is not None and model.carrier(flange).name in arms:
+            way = flange_from_tool[:3, :3] @ tool.tcp.position + flange_from_tool[:3, 3]
+            said = f"between the last joint's axis and the way to the working point of {tool.name}"
+        else:
+            continue
+        beside = np.cross(world_from_flange[:3, 3] - axis[0], axis[1])
+        if np.linalg.norm(beside) > ON_AXIS or np.linalg.norm(way) < ON_AXIS:
+            continue
+        along = abs(float(world_from_flange[:3, :3] @ way @ axis[1])) / float(np.linalg.norm(way))
+        angle = float(np.arccos(min(1.0, along)))
+        yield Quantity(f"tools[{i}].across", "tools.across", "rad", (angle,), (tool.name,), said, tool.name)
+
+
 def _payloads(model: Model) -> Iterator[Quantity]:
     """What hangs on each robot, as a share of what its maker rates it for."""
     for i, robot in enumerate(model.workstation.robots):
@@ -304,6 +337,7 @@ class _Home:
             at = q.get(mechanism.name, mechanism.home)
             data.qpos[mechanism.q_address] = mechanism.coupling @ at + mechanism.offset
         mujoco.mj_kinematics(model.mj, data)
+        self._data = data
         ids = [body.mj for body in model.bodies]
         self.rotations: Array = data.xmat[ids].reshape(-1, 3, 3).copy()
         self.positions: Array = data.xpos[ids].copy()
@@ -315,6 +349,21 @@ class _Home:
             if name in q or (name not in driven and (m.home_given or not m.joints))
         }
         """Robots, people and machines that stand where they are now, as far as the file says."""
+
+    def pose(self, frame: Frame) -> Array:
+        """Where a frame is in the world, shape (4, 4)."""
+        world_from_body = np.eye(4)
+        world_from_body[:3, :3] = self._data.xmat[frame.mj].reshape(3, 3)
+        world_from_body[:3, 3] = self._data.xpos[frame.mj]
+        found: Array = world_from_body @ frame.body_from_frame
+        return found
+
+    def axis(self, model: Model, frame: Frame) -> tuple[Array, Array] | None:
+        """A point and the direction of the axis that a frame turns about; None where it turns about none."""
+        joint = model.mj.body_jntadr[model.mj.body_weldid[frame.mj]]
+        if joint < 0 or model.mj.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
+            return None
+        return self._data.xanchor[joint].copy(), self._data.xaxis[joint].copy()
 
     def lowest(self, bodies: Sequence[Body]) -> float:
         """Height of the lowest point of bodies [m]."""

@@ -43,7 +43,7 @@ FOLLOWS: dict[str, tuple[str, ...]] = {
         "below_floor",
         "stands_on_nothing",
     ),
-    "tools": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart", "tcp_outside"),
+    "tools": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart", "tcp_outside", "across"),
     "workpieces": ("mass", "extent", "bulk_density", "com_outside", "gyration", "apart"),
     "parts": ("extent", "bulk_density", "inside."),
     "areas": ("extent", "below_floor"),

@@ -118,14 +118,15 @@ def test_what_was_imported_is_off_by_as_much_when_a_robot_carries_it(tmp_path, w
     assert 8100 * volume * (1 - 2e-6) <= found.heaviest_load() < 8110 * volume
 
 
-def test_of_a_mass_that_is_spread_nobody_knows_how_only_the_mass_is_written():
+def test_of_a_mass_whose_shape_is_open_the_mass_and_its_even_density_are_written():
     sure = Inertial(2.0, np.zeros(3), np.eye(3), Origin.GIVEN, "file")
     assert _stated_mass(sure).keys() == {"mass", "com", "inertia"}
-    assert _stated_mass(replace(sure, spread_error=0.1)) == {"mass": 2}
+    assert _stated_mass(replace(sure, spread_error=0.1)) == {"mass": 2, "uniform_density": True}
     assert _stated_mass(replace(sure, error=0.1, spread_error=0.1)).keys() == {
         "mass", "mass_tolerance", "com", "inertia",
     }  # fmt: skip
     assert _stated_mass(replace(sure, error=1 / 3, spread_error=0.5)) == {
         "mass": 2,
+        "uniform_density": True,
         "mass_tolerance": 0.333334,
     }

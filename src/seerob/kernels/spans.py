@@ -313,9 +313,9 @@ class Figures(NamedTuple):
     points: Indices
     """Of which Jacobians are, shape (m,)."""
     moves: Flags
-    """As of `column_changes`, shape (m, nv)."""
+    """Which joints count, see `column_changes`, shape (m, nv)."""
     shares: Array
-    """Likewise, 0 in columns that there are not, shape (m, nv, c)."""
+    """The shares of the columns' joints in each joint, 0 in columns that there are not, shape (m, nv, c)."""
 
 
 FIGURES = Layout(
